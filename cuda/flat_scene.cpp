@@ -14,8 +14,7 @@ namespace {
 // area times its number of triangles.
 constexpr int bins = 16;
 constexpr std::size_t most_in_leaf = 4;
-constexpr int deepest_by_area = 32;  // below this depth, items are halved by number; this takes at most 32 more levels
-constexpr float node_cost = 1.2f;    // cost of a node, in triangle tests
+constexpr int deepest_by_area = 32;  // deeper nodes split their items into two equal numbers, in at most 32 more levels
 
 void grow(Box& box, const Box& by) {
   for (int k = 0; k < 3; ++k) {
@@ -28,7 +27,7 @@ float half_area(const Box& b) {
   const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
   return x < 0 ? 0 : x * y + y * z + z * x;
 }
-/// Twice the centre. Only the order and the ratios of centres are used.
+/// Twice the centre. The factor does not matter, because only comparisons and ratios of differences are used.
 float twice_centre(const Box& b, int axis) { return b.low[axis] + b.high[axis]; }
 
 struct Split {
@@ -106,7 +105,8 @@ class Builder {
     if (best.axis < 0) return halve(from, to);
     const auto first = index_.begin() + static_cast<std::ptrdiff_t>(from),
                last = index_.begin() + static_cast<std::ptrdiff_t>(to);
-    // The partition is stable, so that the order of triangles, and the choice between equal hits, is the same in every build.
+    // The partition is stable, so that the order of triangles, and the choice between equal hits, is the same with every
+    // compiler.
     const auto middle =
         std::stable_partition(first, last, [&](std::uint32_t i) { return bin_of(items_[i], centres, best.axis) <= best.bin; });
     return static_cast<std::size_t>(middle - index_.begin());
@@ -116,7 +116,7 @@ class Builder {
     return std::clamp(static_cast<int>(part * bins), 0, bins - 1);
   }
   void consider(std::size_t from, std::size_t to, const Box& centres, int axis, Split& best) const {
-    // If all centres lie in one plane, a split along its normal would divide by a length of 0.
+    // If all centres have the same coordinate on this axis, bin_of() would divide by 0.
     if (!(centres.high[axis] > centres.low[axis])) return;
     std::array<Box, bins> box;
     box.fill(no_box);
@@ -143,7 +143,7 @@ class Builder {
       number += count[b];
       // A plane without items below it does not divide them.
       if (number == 0) continue;
-      const float cost = node_cost + half_area(all) * static_cast<float>(number) + above[b];
+      const float cost = half_area(all) * static_cast<float>(number) + above[b];
       if (cost < best.cost) best = {axis, static_cast<int>(b), cost};
     }
   }
@@ -173,7 +173,7 @@ struct Bounds {
 };
 
 void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std::vector<FlatTriangle>& triangles) {
-  // Computed in double up to the position, then in float relative to the origin of rays [m].
+  // Computed in double, then rounded to float [m]: relative to the origin of rays, or in the axes of a body.
   const Rotation turn = rotation_from(placed.orientation);
   std::vector<std::array<float, 3>> corners;
   corners.reserve(mesh.vertices.size());
@@ -186,7 +186,7 @@ void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std:
     std::copy_n(corners[mesh.triangles[t][0]].begin(), 3, flat.a);
     std::copy_n(corners[mesh.triangles[t][1]].begin(), 3, flat.b);
     std::copy_n(corners[mesh.triangles[t][2]].begin(), 3, flat.c);
-    // Object and triangle of a hit, with the numbers of the scene.
+    // A hit reports the numbers that the scene uses for the object and the triangle.
     flat.object = object;
     flat.triangle = static_cast<std::uint32_t>(t);
     triangles.push_back(flat);
@@ -201,8 +201,8 @@ Box box_of(const FlatTriangle& t) {
   return bounds.box;
 }
 
-/// The box around a rotated body's box. It is slightly larger than necessary, because rays are converted to the body's axes in
-/// float.
+/// The box, in world axes, around a rotated body's own box. It is slightly larger than necessary, because rays are converted to
+/// the body's axes in float.
 Box box_in_world(const Box& own, const PlacedBody& body) {
   Bounds bounds;
   for (int corner = 0; corner < 8; ++corner) {
@@ -214,7 +214,7 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
     bounds.add(at);
   }
   for (int k = 0; k < 3; ++k) {
-    // 1 mm plus the rounding error of float at that distance [m]. A ray that hits the body must also hit the box.
+    // 1 mm plus 1e-5 of the distance, far above the rounding error of float [m]. A ray that hits the body must also hit the box.
     const float slack = 1e-3f + 1e-5f * std::max(std::abs(bounds.box.low[k]), std::abs(bounds.box.high[k]));
     bounds.box.low[k] -= slack;
     bounds.box.high[k] += slack;

@@ -1,5 +1,5 @@
-// The tree of a parsed text, to which Node and Map refer. With this tree, only strict_yaml.cpp needs yaml-cpp. It is internal
-// to core/text; readers use strict_yaml.hpp.
+// The tree of a parsed text, to which Node and Map refer. The tree has no types of yaml-cpp, so that only strict_yaml.cpp
+// includes them. Code outside core/text includes strict_yaml.hpp.
 #pragma once
 
 #include <cstddef>

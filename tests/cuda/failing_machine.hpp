@@ -1,4 +1,4 @@
-// A device that fails at a given call and at all later calls, with host loops inside. Tests use it to examine the consequences.
+// A device for tests of errors: host loops, the device code on the CPU, in which a given call and all later calls fail.
 #pragma once
 
 #include <atomic>
@@ -16,12 +16,13 @@ class FailingMachine final : public cuda::Machine {
  public:
   /// If set, the device has no transforms, for this reason.
   std::string no_transforms;
-  /// Memory of the device [bytes]. A request that exceeds the rest causes DeviceMemoryFull. `tells_bytes` are the free
-  /// bytes that the device reports.
+  /// Memory of the device [bytes]. An allocation beyond what is left throws DeviceMemoryFull. free_bytes() always returns
+  /// `tells_bytes`.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
   /// Simulates an error of the program instead of a lost device: only the call `last` throws std::logic_error.
   bool has_fault = false;
-  /// `calls` counts the calls and must outlive this object. The call number `last` and all later calls fail.
+  /// `calls` counts all calls but releases and queries, and must outlive this object. The calls from number `last` on, counted
+  /// from 0, fail.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}
 
   std::string name() const override { return "a device that fails"; }

@@ -1,5 +1,5 @@
-// Devices with properties of real ones that host loops lack: all work is done as late as the order of lanes allows; threads
-// compute the indices of a step at the same time; pieces of memory are not adjacent.
+// Devices that run on the CPU, with properties of real devices that host loops lack. One does all work as late as the order of
+// lanes allows, one computes the indices of a step in parallel threads, one keeps pieces of memory apart (cuda/machine.hpp).
 #pragma once
 
 #include <array>
@@ -38,12 +38,12 @@ class PassingMachine : public cuda::Machine {
   void wait(int lane) override { inner_->wait(lane); }
 
  protected:
-  // Memory begins as NaN.
+  // With this order new memory is filled with NaN.
   std::unique_ptr<cuda::Machine> inner_ = cuda::make_host_loops(cuda::LoopOrder::backwards);
 };
 
-/// Does no work before a wait for a lane, and then only the work that this lane needs. Sources of copies are read only then. So
-/// a test detects a source that was changed or released too early, and a missing order of lanes.
+/// Does no work before a wait for a lane, and then only the work that this lane needs. A copy reads its source only then. So a
+/// test detects a source that was changed or released too early, and a forgotten call of order().
 class DeferringMachine final : public PassingMachine {
  public:
   void upload(int lane, void* to, const void* from, std::size_t n) override {
@@ -113,7 +113,7 @@ class DeferringMachine final : public PassingMachine {
 };
 
 /// Distributes the indices of a step to four threads. The thread sanitizer then detects two threads that write to one position,
-/// even if the sum is not affected.
+/// even if the result is right.
 class ThreadedMachine final : public PassingMachine {
  public:
   void run(int, const cuda::Launch& launch) override {

@@ -11,7 +11,8 @@
 namespace sonar::render {
 namespace {
 
-/// Returns the values that formulas may use, including those of the sweep. tests/oracles/README.md lists them.
+/// Returns the values that formulas may use, including those of the sweep, without the `first_` ones. tests/oracles/README.md
+/// lists them.
 Values known_values(const RenderJob& job, const PingRequest& request) {
   const FrequencyMode& mode = job.mode();
   const PingSettings& s = job.settings;

@@ -12,9 +12,9 @@ namespace sonar {
 namespace {
 
 constexpr double least_area_m2 = 0.05;
-constexpr double least_width_m = 0.1;        // least area divided by greatest extent; a mirror is many Fresnel zones wide
-constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
-constexpr double same_normal = 1 - 1e-6;     // cosine of the largest angle between normals of one plane
+constexpr double least_width_m = 0.1;        // smallest area divided by greatest extent; narrower faces diffract
+constexpr double same_plane_m = 2e-4;        // width of a bin of offsets: an eighth of a wavelength at 1 MHz
+constexpr double same_normal = 1 - 1e-6;     // cosine of 1.4 mrad; a neighbour whose normal differs by less is coplanar
 constexpr double most_gentle_border = 0.25;  // fraction of the border at gentle bends; above it, the surface is curved
 
 using Triangles = std::vector<std::uint32_t>;
@@ -46,17 +46,17 @@ struct Candidate {
   Triangles triangles;
 };
 
-/// Collects coplanar triangles. Planes are sorted into bins by rounded numbers. If a plane is close to the border of its bin,
-/// the neighbouring bin is searched, too.
+/// Collects coplanar triangles of one material. Bins are rounded normals and offsets. If a plane is close to a border of its bin,
+/// the bins beyond that border are searched, too.
 class FaceSorter {
  public:
   void add(const Mesh& mesh, std::uint32_t t) {
-    // Keeps the plane of the largest triangle so far, because its rounding error is smallest.
     const Vec3d twice = area_vector(mesh, t);
     const double area = 0.5 * length(twice);
     if (!(area > 0)) return;
     const Vec3d n = one_sided((0.5 / area) * twice);
     Candidate& c = candidate_of({n, dot(n, corner(mesh, t, 0))}, mesh.material[t]);
+    // The plane of the largest triangle has the smallest rounding error.
     if (area > c.largest_m2) c.plane = {n, dot(n, corner(mesh, t, 0))}, c.largest_m2 = area;
     c.material = mesh.material[t];
     c.area_m2 += area;
@@ -144,7 +144,7 @@ bool curves_on(const Mesh& mesh, const Edges& edges, const Candidate& c) {
         const Vec3d n = area_vector(mesh, other);
         cosine = std::max(cosine, std::abs(dot(n, c.plane.normal)) / std::max(length(n), 1e-30));
       }
-      if (cosine > same_normal) continue;  // inside the face
+      if (cosine > same_normal) continue;  // a coplanar neighbour: no border
       border_m += length(to - from);
       if (cosine > gentle_bend) gentle_m += length(to - from);
     }

@@ -21,12 +21,12 @@ namespace sonar {
 
 class MavlinkServer {
  public:
-  /// Links and origin are read from `config` now; the allowed addresses are read for each datagram. `began`: the daemon's time
-  /// that counts as boot time in messages.
+  /// `config` must outlive the object: open() reads the links and the geographic origin, and each datagram the allowed addresses.
+  /// `began`: the daemon's time from which messages count the time since boot.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log, Time began);
 
-  /// Call it before open(). Sets the function for the command to inject a failure, on every link. Without the function the answer
-  /// to the command is "unsupported".
+  /// Call it before open(). Sets the function, for all links, that carries out the command to inject a failure. Without the
+  /// function the answer to the command is "unsupported".
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   /// Call it before open(). `tell` is called when wants_distances() of a vehicle has changed.
   void on_distances_wanted(std::function<void()> tell) { distances_wanted_ = std::move(tell); }
@@ -40,9 +40,9 @@ class MavlinkServer {
 
   /// Returns texts such as "udpin:127.0.0.1:14551", with the port that the system chose for 0.
   std::vector<std::string> endpoints() const;
-  /// Returns the counts of the distances of each link, in the order of the configuration.
+  /// Returns for each link how many distances were sent and dropped, in the order of the configuration.
   std::vector<LinkFigures> figures() const;
-  /// Returns notes that list the missing messages of links without poses.
+  /// Returns notes on links without poses, with the missing messages, and on ignored messages of a second system.
   std::vector<Note> notes() const;
   /// Returns the address of a listening link; links are in the order of the configuration.
   Endpoint listens_at(std::size_t link) const;
@@ -55,7 +55,7 @@ class MavlinkServer {
     mavlink::MavlinkPoses poses;
     udp::socket socket;
     asio::steady_timer timer;
-    std::optional<udp::endpoint> peer;  // the address to which replies are sent
+    std::optional<udp::endpoint> peer;  // gets heartbeats, requests and distances; a reply goes to the sender of its request
     std::string name;                   // such as "mavlink udpin:127.0.0.1:14551"
     LogLimiter notices = {}, drops = {};
     LinkFigures distances = {};
