@@ -30,7 +30,7 @@ tl::unexpected<Error> not_opened(const std::filesystem::path& file) {
   const std::string why = error == ELOOP    ? "its links lead round in a circle, or are too many; name the file itself"
                           : error == EACCES ? "Permission denied; give this user the right to read it and to enter its folders"
                           : to.empty()      ? std::strerror(error)
-                                            : "it is a link to " + to + ", which is not there";
+                                            : "it is a link to \"" + to + "\", which does not exist";
   return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + why);
 }
 

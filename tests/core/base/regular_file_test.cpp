@@ -51,7 +51,7 @@ TEST_F(RegularFile, LinksThatLeadToNoFileAreExplained) {
   std::filesystem::create_symlink("round", folder / "round");
   std::filesystem::create_symlink("gone", folder / "link");
   EXPECT_THAT(refusal(folder / "round"), HasSubstr("round: cannot be opened: its links lead round in a circle, or are too many"));
-  EXPECT_THAT(refusal(folder / "link"), HasSubstr("link: cannot be opened: it is a link to gone, which is not there"));
+  EXPECT_THAT(refusal(folder / "link"), HasSubstr("link: cannot be opened: it is a link to \"gone\", which does not exist"));
   EXPECT_THAT(refusal(folder), HasSubstr("; name a file in it"));
   for (const char* name : {"round", "link", "."}) EXPECT_FALSE(is_absent(folder / name)) << name;
   EXPECT_TRUE(is_absent(folder / "none"));

@@ -39,10 +39,10 @@ const std::string sonar = "sonars:\n  - name: front\n    profile: oculus-m1200d\
 
 TEST(ConfigMistakes, NamesTheNearestSceneForAnUnknownName) {
   std::ofstream(directory() + "/harbour.yaml") << "objects: []\n";
-  std::ofstream(directory() + "/harbours.yaml") << "world: {scene: harbour.yaml}\nobjects: []\nsonars: []\n";  // no scene
+  std::ofstream(directory() + "/harbours.yaml") << "world: {scene: harbour.yaml}\nobjects: []\nsonars: []\n";  // not a scene
   const auto refusal = [&](const std::string& scene) { return why("world: {scene: " + scene + "}\n" + vehicles + sonar); };
   EXPECT_THAT(refusal("harbuors.yaml"), HasSubstr("no such file: \"harbuors.yaml\"; did you mean \"harbour.yaml\"? Looked in "));
-  EXPECT_THAT(refusal("demoo.yaml"), HasSubstr("did you mean \"demo.yaml\"?"));  // part of the program
+  EXPECT_THAT(refusal("demoo.yaml"), HasSubstr("did you mean \"demo.yaml\"?"));  // a built-in scene
   EXPECT_THAT(refusal("local-search"), HasSubstr("did you mean \"local-search.yaml\"?"));
   EXPECT_THAT(refusal("scenes/demo.yml"), HasSubstr("did you mean \"demo.yaml\"?"));
 }
@@ -61,7 +61,7 @@ TEST(ConfigMistakes, SaysWhyAnExistingFileCannotBeRead) {
   const std::pair<const char*, const char*> cases[] = {
       {"maps.yaml", "maps.yaml: is a folder, not a regular file; name a file in it"},
       {"round.yaml", "round.yaml: cannot be opened: its links lead round in a circle"},
-      {"link.yaml", "link.yaml: cannot be opened: it is a link to gone, which is not there"}};
+      {"link.yaml", "link.yaml: cannot be opened: it is a link to \"gone\", which does not exist"}};
   for (const auto& [name, words] : cases) {
     EXPECT_THAT(why(std::string("world: {scene: ") + name + "}\n" + vehicles + sonar), HasSubstr(words));
     EXPECT_THAT(why(world + "vehicles: [{name: a, trajectory: {file: " + name + "}}]\n" + sonar), HasSubstr(words));
@@ -148,7 +148,7 @@ TEST(ConfigMistakes, UnknownOptionsAreRefusedWithTheKnownOnes) {
   EXPECT_THAT(with("before_frist_fire: pings"),
               ::testing::AllOf(HasSubstr("sonars[0].options.before_frist_fire: unknown key"), HasSubstr("heads_base")));
   EXPECT_THAT(with("strict_rnage: on"), HasSubstr("did you mean \"strict_range\"?"));
-  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // a key that is also in the wrong section
+  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // an option of another make
 }
 
 TEST(ConfigMistakes, TheDemoAcceptsAnyProduct) {
