@@ -1,5 +1,5 @@
-// Compares an M3 with the published layout: bytes at the offsets of the tables, samples, windows of real packets, and how its
-// host decodes packets that this file builds without our writer.
+// Compares the emulated M3 with the published layout (bytes at the offsets of its tables) and with the sampling windows of real
+// packets, and its host with packets that this file builds without our writer.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ protocol::DeviceState device(const char* positive_angles = "port") {
 
 constexpr std::size_t beams = 128;
 
-/// Returns a ping without signals. In samples that set() writes, the code 2^22 is an amplitude of 1.
+/// Returns a ping of zeros. In samples that set() writes, the code 2^22 is an amplitude of 1.
 Ping ping_of(const protocol::DeviceState& state, const Settings& settings = {}) {
   Ping ping;
   PingRequest& r = ping.request;
