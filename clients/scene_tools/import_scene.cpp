@@ -95,7 +95,7 @@ bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {
   return true;
 }
 
-/// The suffix gives the format; the daemon's loader checks the rest.
+/// Returns why a mesh cannot be used: its suffix is unknown, or the daemon's loader refuses it.
 std::string FileResolver::why_not(const fs::path& file) {
   static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
   if (std::find(known.begin(), known.end(), mesh_extension(file)) == known.end())
@@ -238,7 +238,8 @@ class MaterialChooser {
     return chooser;
   }
 
-  /// Chooses a material from names in the files: of the appearance, the shape, the model, and the file or library of the model.
+  /// Chooses a material: that of --material, else by words in the names of appearance, shape, link, model and mesh, else a
+  /// default.
   std::string choose(const PlacedShape& shape, const ImportedModel& model) const {
     for (const auto& [path, name] : for_model_)
       if (model.path == path || model.path.starts_with(path + "/")) return name;

@@ -73,7 +73,7 @@ class Findings {
   void leave_out(const Place& at, const std::string& what);  // lists each place and sentence once
   /// Counts an omitted element, such as a "light". The names of models, if any, are listed with the count.
   void leave_out_of_no_echo(const std::string& kind, std::string_view name = {});
-  /// Lists a file that is named but not found, once, with the number of times. `fetch`: the command that fetches it; may be
+  /// Lists a missing file once, with the number of references to it. `fetch`: the command that fetches it; may be
   /// empty. Files that the same command fetches are listed once.
   void leave_out_missing(const Place& at, const std::string& what, const std::string& fetch, std::size_t times = 1);
   bool failed() const { return error_.has_value(); }
@@ -85,7 +85,7 @@ class Findings {
   std::optional<Error> error_;
   std::vector<std::string> left_out_;
   struct Missing {
-    std::string place, what, fetch;  // those of the first
+    std::string place, what, fetch;  // those of the first missing file
     std::size_t times = 0;
     std::set<std::string> names = {};
   };

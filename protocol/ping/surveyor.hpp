@@ -20,7 +20,7 @@ struct Settings {
 };
 /// Compares settings; clock offsets that differ by less than a millisecond count as equal.
 bool same_settings(const Settings& a, const Settings& b);
-/// Returns the detected points of the ping, as a std::vector<Detection>.
+/// Returns the detected points of the ping; they hold a std::vector<Detection>.
 std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);
 using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.

@@ -1,4 +1,5 @@
-"""Measures the memory of a daemon with a sonar of every make while clients send mutated messages to all ports. Run by hand:
+"""Measures the memory of a daemon with a sonar of every make while clients send mutated messages to one port of each.
+Run by hand:
 build/release/tests/own_network/in_own_network python3 tests/load/mutated_messages.py [SECONDS]
 
 Many of the messages are valid and change settings, so that the tables for settings and the cells of the scene fill up to their

@@ -27,7 +27,7 @@ class Audience {
   bool has_audience() const { return connections_.has_audience(); }
   bool stopping() const { return stopping_; }
 
-  /// Admits a new connection if a slot is free, unless a fault of clients (`by_fault`) changes the verdict. Returns the
+  /// Admits a new connection if a slot is free, unless an injected fault (`by_fault`) decides otherwise. Returns the
   /// connection if it gets a slot (the caller must then call serve()); null if it waits or is refused. After a take-over the
   /// previous client no longer counts as a client.
   Connection* admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
@@ -41,15 +41,16 @@ class Audience {
   void hand_over(ConnectionId id, Peer to);
   /// Sets the list of receivers of client `from`, or of the device if `from` is null. An address 0.0.0.0 becomes `ip`.
   void set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted);
-  /// Restores the device's own list of a stream to that of the stored configuration.
+  /// Replaces the device's own list of a stream by `initial`.
   void restore_receivers(protocol::SetReceivers initial);
   /// Call it after a client has connected or left: updates the client in status messages, and drops pings without receivers.
   void on_membership();
 
-  /// Ends a connection: drops waiting pings, but still sends the current message and replies.
+  /// Marks a connection as ending, and drops its waiting pings; the current message and replies stay in the outbox.
   void finish(Connection& connection);
+  /// Like finish(), and tells the caller to close the connection after these.
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
-  /// Ends all connections as finish() does, and admits no more.
+  /// Resets waiting connections, ends the others as begin_finish() does, and admits no more.
   void stop(const std::string& why, Actions& actions);
   /// Adds the counts of a closed connection to the figures, and removes the connection.
   void remove(Connection& connection, const std::string& why, bool by_client, Actions& actions);

@@ -96,7 +96,7 @@ bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   return false;
 }
 
-/// True for the descriptors just below the reserved ones, which are for drivers.
+/// True for the descriptors that are kept for drivers, and for higher ones.
 bool Admission::is_drivers(const tcp::socket& socket) const {
   const std::uint64_t for_drivers = std::min(most_kept_for_drivers, most_descriptors() / 8);
   return number_of(socket) >= first_spare(limits_, Purpose::client) - for_drivers;

@@ -93,7 +93,7 @@ TEST(Fan, ShowsNothingNearerThanItsStart) {
   EXPECT_EQ(grey_at(5.1).b, 50);
 }
 
-/// One step from the last bearing leads to the first one, as for a head that keeps turning.
+/// Returns an image with beams all around: the last bearing is one step from the first, as for a head that keeps turning.
 PolarImage full_turn(std::size_t beams, double first_rad) {
   PolarImage image = black_fan(10, beams, 180);
   for (std::size_t i = 0; i < beams; ++i)
@@ -114,9 +114,9 @@ TEST(Fan, AFullTurnHasNoGap) {
     }
   }
   PolarImage gap = full_turn(16, pi);
-  for (double& azimuth : gap.azimuth_rad) azimuth *= 0.9;  // 36 degrees are missing, minus the half beams
+  for (double& azimuth : gap.azimuth_rad) azimuth *= 0.9;  // 56 degrees without a bearing, 36 without a beam
   const Raster fan = *draw_fan(gap, plain_gray());
-  EXPECT_EQ(fan.at(195, fan.height - 10).b, outside_colour.b) << "a sector stays one";
+  EXPECT_EQ(fan.at(195, fan.height - 10).b, outside_colour.b) << "a sector is not closed to a circle";
 }
 
 TEST(Fan, KeepsTheMeanWhenPixelsAreCoarserThanSamples) {
